@@ -34,7 +34,6 @@ from dolfinx_contact.problem_input import (
     checked_contacts,
     checked_form_options,
     checked_internal,
-    checked_lagged,
     checked_options,
     checked_solver,
     checked_tolerance,
@@ -43,6 +42,7 @@ from dolfinx_contact.problem_input import (
     multigrid_is_faster,
     support,
     take_contacts,
+    validated_lagged,
 )
 from dolfinx_contact.results.record import (
     NO_SOLUTION,
@@ -152,7 +152,7 @@ class ContactProblem(Guarded):
         tol=checked_tolerance,
         geometry_tol=partial(positive, "geometry_tol"),
         undetermined=checked_undetermined,
-        lagged=checked_lagged,
+        lagged=validated_lagged,
         checks=checked_checks,
     )
     _settable = ("bcs", "monitor", *_checked)

@@ -216,7 +216,7 @@ def multigrid_is_faster(solver: Solver, body: ElasticBody, contacts: Sequence[Co
     return isinstance(solver, (Automatic, FixedPoint)) and nodes > most
 
 
-def checked_lagged(quantities: Any) -> tuple:
+def validated_lagged(quantities: Any) -> tuple:
     """Return the user's lagged quantities as a tuple.
 
     Raises:

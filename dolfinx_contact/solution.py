@@ -59,7 +59,7 @@ def solution(problem: ContactProblem) -> tuple[SolverResult, dict, str]:
 def _levels(problem: ContactProblem, step: LoadStep) -> list:
     """Return the lagged quantities of the step by levels, the innermost loop first.  Collective."""
     contacts, levels = problem.contacts, []
-    if any(contact.laws.follow_pressure for contact in contacts):
+    if any(contact.laws.depends_on_pressure for contact in contacts):
         from dolfinx_contact.lagged.friction import PressureFriction
 
         levels.append([PressureFriction()])

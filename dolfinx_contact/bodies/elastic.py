@@ -19,10 +19,10 @@ from petsc4py import PETSc
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.input import (
-    agree_on_values,
     check_diagonal,
     check_dilation,
     check_finite,
+    check_same_values,
     digest_of,
     same_values,
     values_of,
@@ -169,7 +169,7 @@ class ElasticBody(OverRanks):
             Number of assemblies so far, which identifies the matrix.
         """
         given = *self._parameters, *self._load_parameters, *compat.bc_constants(self.bcs)
-        agree_on_values(given, self.comm)
+        check_same_values(given, self.comm)
         fixed = self._digest is not None and np.array_equal(self.fixed, self._assembled_fixed)
         if self._all_same(fixed and same_values(self._parameters, self._assembled_with)):
             return self.assemblies

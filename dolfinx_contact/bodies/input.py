@@ -157,7 +157,7 @@ def check_dilation(body: ElasticBody) -> None:
         )
 
 
-def agree_on_values(parameters: Iterable[Any], comm: MPI.Comm) -> None:
+def check_same_values(parameters: Iterable[Any], comm: MPI.Comm) -> None:
     """Raise a ``ValueError`` on all ranks if a constant differs between ranks.  Collective.
 
     Ghost values of Functions are updated.

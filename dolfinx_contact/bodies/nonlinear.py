@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx_contact import compat
 from dolfinx_contact.bodies import rigid_motion
 from dolfinx_contact.bodies.elastic import ElasticBody
-from dolfinx_contact.bodies.input import agree_on_values, check_diagonal, check_finite
+from dolfinx_contact.bodies.input import check_diagonal, check_finite, check_same_values
 from dolfinx_contact.petsc.linear_solver import preconditioner
 from dolfinx_contact.support.collective import raised_together
 
@@ -107,7 +107,7 @@ class NonlinearBody(ElasticBody):
         Raises:
             ValueError: a rigid motion of the body is unsupported, or the stiffness is not positive.
         """
-        agree_on_values((*self._given, *compat.bc_constants(self.bcs)), self.comm)
+        check_same_values((*self._given, *compat.bc_constants(self.bcs)), self.comm)
         if x is not None:
             self._place = self._rounding = None  # constants and coefficients may have changed
             self.linearise(x)

@@ -163,7 +163,7 @@ class ContactStep:
             slip[:, :-1] -= self.before
         known = points.known(slip, (motion, moved, self.last.displacement))
         slip = slip[:, :-1]
-        points.without_held(slip)
+        points.remove_constrained(slip)
         if known is not None:
             slip += known
         slip[points.alone] = 0.0  # facing no surface

@@ -54,7 +54,7 @@ def dragged(contact: ContactStep, state: State, missed: np.ndarray) -> np.ndarra
         state: State at the end of the step.
         missed: Errors of the slips, ``shape=(n, gdim - 1)``, local frame, length; changed in place.
     """
-    contact.points.without_held(missed)
+    contact.points.remove_constrained(missed)
     made = np.linalg.norm(np.einsum("nij,nj->ni", contact.stiffness.tangential, missed), axis=1)
     # The direction of friction of a slipping node changes at most as much as that of its slip.
     slip = np.linalg.norm(state.slip_increment, axis=1)
@@ -137,7 +137,7 @@ def _turn_along_path(
     bends = np.linalg.norm(np.diff(normals, axis=0), axis=2)
     bends[np.isnan(bends)] = np.pi  # through a place without a normal, such as a centre
     if dim == 3:  # and about the normal
-        turned = geometry.turned_to(surface, contact.given.history)
+        turned = geometry.rotation_since_last_step(surface, contact.given.history)
         bends = np.hypot(bends, (normals[-1] @ turned) / PLACES_ON_WAY)
     within = touched & opens
     return np.concatenate((np.zeros((1, count)), np.cumsum(np.where(within, bends, 0.0), axis=0)))
@@ -162,7 +162,7 @@ def _path(
     The array has ``shape=(PLACES_ON_WAY + 1, n, gdim)``.  In space, nodes move on straight lines,
     and the surface moves and rotates uniformly.
     """
-    turned = geometry.turned_to(surface, history)
+    turned = geometry.rotation_since_last_step(surface, history)
     start, end = geometry.started(history) - surface.point, end - surface.point
     parts = np.linspace(0.0, 1.0, PLACES_ON_WAY + 1)
     if not turned.any():

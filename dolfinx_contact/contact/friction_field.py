@@ -116,7 +116,7 @@ def _coefficients(contact: Contact, name: str, given: Any, state: dict[str, np.n
     return np.broadcast_to(values, (2, n)).T.copy()
 
 
-def wear_on_nodes(contact: Contact, wear: Wear | None) -> np.ndarray | None:
+def nodal_wear_coefficients(contact: Contact, wear: Wear | None) -> np.ndarray | None:
     """Wear coefficients at each owned node, ``shape=(n, 2)``; None without a wear field.
 
     Raises:

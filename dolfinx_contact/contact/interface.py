@@ -151,7 +151,7 @@ class ContactPoints:
         known[self.supported] = part
         return None if still.all() else known
 
-    def without_held(self, tangential: np.ndarray) -> None:
+    def remove_constrained(self, tangential: np.ndarray) -> None:
         """Remove the constrained parts from tangential vectors, in place.
 
         Args:

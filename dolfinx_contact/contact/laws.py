@@ -78,7 +78,7 @@ class Laws:
         field = None
         with raised_together(contact.comm):
             if wear is not None:
-                field = _friction_field().wear_on_nodes(contact, wear)
+                field = _friction_field().nodal_wear_coefficients(contact, wear)
         self.wear, self.wear_field = wear, field
 
     def _evaluated_friction(
@@ -173,7 +173,7 @@ class Laws:
         return np.abs(new[:, 0] * axes[:, 1] - new[:, 1] * axes[:, 0])
 
     @property
-    def follow_pressure(self) -> bool:
+    def depends_on_pressure(self) -> bool:
         """Whether friction depends on the contact pressure at the end of the step."""
         return self._field is not None and "pressure" in _friction_field().followed(self._field)
 
@@ -200,7 +200,7 @@ class Laws:
             before: The present law, which is returned if its coefficients do not change.
             frames: Frames of the nodes.
         """
-        if not self.follow_pressure:
+        if not self.depends_on_pressure:
             return before
         given = dict(axes=before.axes, pressure=pressure, frames=frames)
         friction = self._evaluated_friction(contact, self._field, **given)

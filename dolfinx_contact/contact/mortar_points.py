@@ -282,7 +282,7 @@ class MortarGeometry(NodalGeometry):
         slip = before.points.motion(u - frames.start)
         slip[:, -1] = 0.0
         slip = times(frames.frame, to_global(before.frame, slip))[:, :-1]
-        frames.points.without_held(slip)
+        frames.points.remove_constrained(slip)
         return alone & ~before.points.alone, slip
 
     def saved_at(self, at: np.ndarray | None, before: Frames) -> Frames:

@@ -154,7 +154,7 @@ class RigidGeometry(NodalGeometry):
 
     # -- the way of a step ---------------------------------------------------------------------
 
-    def turned_to(self, surface: Surface, history: History) -> np.ndarray:
+    def rotation_since_last_step(self, surface: Surface, history: History) -> np.ndarray:
         """Return the rotation of a surface since the last step, in its axes, radians.
 
         It is a rotation vector, in 2-D an angle.
@@ -187,7 +187,7 @@ class RigidGeometry(NodalGeometry):
         began = self.started(history)
         n1, n0 = own[..., -1, :], surface.frames(began)[..., -1, :]
         chord = y - began - distance[:, None] * n1 + history.last.gap[:, None] * n0
-        way = _round(chord, n0, n1, self.turned_to(surface, history))
+        way = _round(chord, n0, n1, self.rotation_since_last_step(surface, history))
         return times(own[..., :-1, :], way - (y - began))
 
     def started(self, history: History) -> np.ndarray:

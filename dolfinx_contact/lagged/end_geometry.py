@@ -74,7 +74,7 @@ class EndGeometry(Lagged):
         return self._step_at(step, self._ends.after(state.x))
 
     def not_settled(self, change: Change) -> str:
-        return undivided(change.size, self._tol, self._repeated)
+        return geometry_error_message(change.size, self._tol, self._repeated)
 
 
 class Ends:
@@ -177,7 +177,7 @@ def too_long(state: StepState) -> str:
     return f"the step is too long: {message}. Divide the step, or let dc.advance do so"
 
 
-def undivided(missed: float, tol: float, repeated: int) -> str:
+def geometry_error_message(missed: float, tol: float, repeated: int) -> str:
     """Return the error message for a step whose geometry has not converged.
 
     Args:

@@ -121,7 +121,7 @@ def _friction_change(
     step, squares = state.step, 0.0
     for contact, nodes, slip, here in zip(step.contacts, state.nodes, slips, at):
         slip = np.where(here[:, None], slip, 0.0)
-        contact.points.without_held(slip)
+        contact.points.remove_constrained(slip)
         made = np.linalg.norm(np.einsum("nij,nj->ni", contact.stiffness.tangential, slip), axis=1)
         most = 2.0 * contact.friction.mu.max(axis=-1) * nodes.reaction[:, -1]
         squares += np.square(np.minimum(made, most)[here]).sum()

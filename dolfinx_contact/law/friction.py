@@ -388,7 +388,7 @@ class Friction(Guarded):
         mu = np.broadcast_to(self.mu[..., : t.shape[1]], t.shape)
         return np.divide(self.along_axes(t), mu, out=np.zeros_like(t), where=mu > 0)
 
-    def along_radii(self, t: np.ndarray) -> np.ndarray:
+    def times_radii(self, t: np.ndarray) -> np.ndarray:
         """``M t`` for tangential vectors ``t`` in the local frame, ``shape=(n, T)``, same frame."""
         return self._from_axes(self.mu[..., : t.shape[1]] * self.along_axes(t))
 

@@ -25,7 +25,7 @@ from dolfinx_contact.contact.saved import check_saved, load_saved, saved_of
 from dolfinx_contact.contact.state import OPPOSITE_WEAR
 from dolfinx_contact.support.checks import number
 from dolfinx_contact.support.collective import raised_together
-from dolfinx_contact.support.numbering import original_cells, original_nodes
+from dolfinx_contact.support.numbering import original_cells, original_node_numbers
 
 if TYPE_CHECKING:
     from dolfinx_contact.contact.contact import Contact
@@ -400,7 +400,7 @@ def _nodes(body: ElasticBody, contacts: Sequence[Contact]) -> dict[str, np.ndarr
 
     For mixed spaces, the original indices of the cells are included.
     """
-    original = original_nodes(body.displacements.V)
+    original = original_node_numbers(body.displacements.V)
     of_contacts = {f"contact{k}_nodes": original[c.nodes] for k, c in enumerate(contacts)}
     if body.displacements.mixed:
         with raised_together(body.comm):

@@ -108,7 +108,7 @@ class Search:
         change = errors.change * self._contraction()
         within = self.error <= tol  # only then is the forward error part of the rank
         rank = (not within, max(self.error, change) if within else self.error)
-        strays = not errors.acts and self.step.was_pressed
+        strays = not errors.acts and self.step.was_held_by_contact
         if rank < self._rank and not strays:
             self._rank, self.best, self.forward_error = rank, state, change
         if rank < self._attempt and not strays:

@@ -149,7 +149,7 @@ class LoadStep:
         return bool(self.body.comm.allreduce(any(may)))
 
     @cached_property
-    def was_pressed(self) -> bool:
+    def was_held_by_contact(self) -> bool:
         """Whether contact alone holds the body and did so at the last step's end.  Collective."""
         if self.statics is None:
             return False
@@ -157,7 +157,7 @@ class LoadStep:
         return self.body.largest(np.concatenate(pressed)) > 0.0
 
     @cached_property
-    def measuring_maps(self) -> list[NodalMap]:
+    def error_maps(self) -> list[NodalMap]:
         """The return map of each contact, by which errors of states are measured."""
         return [contact.measuring_map() for contact in self.contacts]
 
@@ -219,7 +219,7 @@ class LoadStep:
         insensitive to rounding in the forces.  For arguments see ``evaluate``.
         """
         given: dict[str, Any] = dict(forces=self.residual_forces(x), c=c, before=before, near=near)
-        return self.evaluate(x, self.measuring_maps, exact=True, **given)
+        return self.evaluate(x, self.error_maps, exact=True, **given)
 
     def open(self, x: np.ndarray, c: np.ndarray | None = None) -> StepState:
         """Return the state at a displacement with zero reactions, with forces by F.  Collective."""
@@ -376,9 +376,9 @@ class LoadStep:
             guesses = [*([] if away else guesses), self.statics.start.copy()]
         for guess in guesses:
             guess[self.body.fixed] = self.b[self.body.fixed]
-        states = [self.evaluate(guess, self.measuring_maps) for guess in guesses]
+        states = [self.evaluate(guess, self.error_maps) for guess in guesses]
         # Without acting forces, errors are not relative to forces: such states come last.
-        strays = [self.was_pressed and not state.balance.acts for state in states]
+        strays = [self.was_held_by_contact and not state.balance.acts for state in states]
         return min(zip(strays, states), key=lambda both: (both[0], both[1].balance.error))[1]
 
     # -- errors and messages -------------------------------------------------------------------
@@ -406,7 +406,11 @@ class LoadStep:
         left, acting = state.residual + body.cancelling(self.missing(x)), np.abs(self.external)
         for contact, nodes in zip(self.contacts, state.nodes):
             contact.points.add_magnitudes(nodes.reaction, acting)
-        change = np.full(1, np.inf) if state.acts_before is None else state.acts - state.acts_before
+        change = (
+            np.full(1, np.inf)
+            if state.previous_reactions is None
+            else state.acts - state.previous_reactions
+        )
         cancelling = UNIT_ROUNDOFF * (body.cancelling(x) + acting)
         if self.surfaces is not None:
             on_surfaces, terms = self.surfaces.left(state.nodes, state.c)
@@ -476,7 +480,7 @@ class LoadStep:
         """Return a message on why the step has not converged, and what may help.  Collective."""
         message = "" if self.statics is None else self.statics.hidden(self)
         message = message or self._reason_without_state(state) or self._advice()
-        if any(contact.given.laws.follow_pressure for contact in self.contacts):
+        if any(contact.given.laws.depends_on_pressure for contact in self.contacts):
             message += "; friction follows the pressure, and was that of the last iterate"
         if any(contact.given.laws.wears_within for contact in self.contacts):
             message += (
@@ -566,7 +570,7 @@ class StepState:
         return replace(self, is_start=True)
 
     @property
-    def acts_before(self) -> np.ndarray | None:
+    def previous_reactions(self) -> np.ndarray | None:
         """Reactions ``acts`` of the previous state; None if unknown."""
         return None if self.before is None else self.before[0]
 

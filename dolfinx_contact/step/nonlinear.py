@@ -33,7 +33,7 @@ class NonlinearStep(LoadStep):
         for guess in self.starts:
             if any(self.body.same(guess, other.x) for other in different):
                 continue
-            state = self.evaluate(guess, self.measuring_maps)
+            state = self.evaluate(guess, self.error_maps)
             left = self.with_reactions(state.forces, state.nodes)
             sizes.append(self.size(left - self.body.carried(self.missing(guess))))
             different.append(state)

@@ -88,7 +88,7 @@ class Statics:
         for contact in contacts:
             points = contact.points
             motion = points.motion(self._modes)
-            points.without_held(motion[:, :-1])
+            points.remove_constrained(motion[:, :-1])
             motion[points.closed] = 0.0
             turns = principal_axes(contact.free_friction, points.count, self._dim)
             parts.append(turns @ motion)

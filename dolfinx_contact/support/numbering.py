@@ -32,7 +32,7 @@ def original_cells(mesh: Mesh) -> np.ndarray:
     return np.array(known[:count], dtype=np.int64)
 
 
-def original_nodes(V: fem.FunctionSpace) -> np.ndarray:
+def original_node_numbers(V: fem.FunctionSpace) -> np.ndarray:
     """Return a number of each owned node that does not depend on the partition of the mesh.
 
     For a vertex, it is the vertex's index in the mesh as it was read or created.  The node of an

@@ -411,7 +411,7 @@ def _unconstrained_columns(contact: ContactStep, columns: np.ndarray) -> np.ndar
     Rows of nodes whose normal displacement is prescribed are zero.
     """
     points, axes = contact.points, columns.copy()
-    points.without_held(axes[:, :-1])
+    points.remove_constrained(axes[:, :-1])
     if contact.dragged is not None:
         rows = contact.dragged.any(axis=1)
         axes[rows, :-1] = columns[rows, :-1]

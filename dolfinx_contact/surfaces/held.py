@@ -225,7 +225,7 @@ class HeldSurface:
         for k, rows, axes in self._holding:
             law, R = contacts[k].friction.at(rows), nodes[k].reaction[rows, -1]
             if axes.shape[1] == axes.shape[2] == 2:
-                parts = [law.along_radii(axis) for axis in np.moveaxis(axes, 2, 0)]
+                parts = [law.times_radii(axis) for axis in np.moveaxis(axes, 2, 0)]
             else:
                 parts = [law.drag(axis) for axis in np.moveaxis(axes, 2, 0)]
             most.append(R[:, None, None] * np.stack(parts, axis=2))

@@ -291,7 +291,7 @@ def test_derivatives_at_shared_nodes_are_those_of_differences():
     for array in (x, way):
         array[body.fixed] = 0.0
     x[body.fixed] = step.b[body.fixed]
-    maps = step.measuring_maps
+    maps = step.error_maps
 
     def left(at):
         return step.evaluate(at, maps).residual - step.free(step.forces(at))

@@ -78,8 +78,8 @@ def test_evaluations_of_foreign_displacements_change_nothing(name, monkeypatch):
         for _ in range(FOREIGN):
             x = found.x + size * random.normal(size=found.x.size)
             with np.errstate(all="ignore"):
-                other = step.evaluate(x, step.measuring_maps, before=found)
-                step.derivatives(other, step.measuring_maps)
+                other = step.evaluate(x, step.error_maps, before=found)
+                step.derivatives(other, step.error_maps)
                 asked.append(other.errors.largest)
         after = held(step, found)
         assert len(before) == len(after) > 20

@@ -426,5 +426,5 @@ def test_half_the_way_of_a_step():
     half = half_step(scene.problem.load_step())
     scene.problem.solve()
     mean = 0.5 * (before + scene.u.x.array[: scene.problem.body.size])
-    state = half.evaluate(mean, half.measuring_maps)
+    state = half.evaluate(mean, half.error_maps)
     assert half.held(mean) and half.size(state.residual) <= 1e-9 * half.scale(state)

@@ -240,7 +240,7 @@ class BoundFixedPoint(BoundSolver):
                 yield "soft motions", factor, TANGENT_INTERVAL
             for every, where in again:
                 if where == FROM_START:
-                    begin(step.evaluate(x, step.measuring_maps, c=c).as_start)
+                    begin(step.evaluate(x, step.error_maps, c=c).as_start)
                 elif where == HALF_WAY:
                     begin(self._half_way(search, factor))
                 else:
@@ -263,7 +263,7 @@ class BoundFixedPoint(BoundSolver):
         search.count(other.iterations)
         x = other.nearest.x.copy()
         x[step.body.fixed] = step.b[step.body.fixed]
-        return step.evaluate(x, step.measuring_maps, c=other.nearest.c)
+        return step.evaluate(x, step.error_maps, c=other.nearest.c)
 
     def _fall(self, search: Search, factor: float, every: int) -> None:
         """Iterate with Anderson acceleration and one ``rho`` until the present attempt ends.
@@ -303,7 +303,7 @@ class BoundFixedPoint(BoundSolver):
                 useless = search.error > USELESS_TANGENT * tangent
                 # keep a tangent that reduced the error by more than the reduction still needed
                 if useless or tangent == np.inf or search.error**2 > step.tol * tangent:
-                    self.preconditioner.forget_tangent()
+                    self.preconditioner.use_springs_only()
                     if not useless:
                         self.preconditioner.linearise(step, step.derivatives(state, maps))
                     anderson.restart()
@@ -333,5 +333,5 @@ class BoundFixedPoint(BoundSolver):
             self.preconditioner = ContactPreconditioner(step, maps)
             self._factor = factor
         if not known:
-            self.preconditioner.forget_tangent()
+            self.preconditioner.use_springs_only()
         return maps

@@ -115,7 +115,7 @@ class ContactPreconditioner:
             self._layer.linearise(step, derivatives)
         self.linearised = True
 
-    def forget_tangent(self) -> None:
+    def use_springs_only(self) -> None:
         """Stop using the contact tangent: corrections use the springs only."""
         self.linearised = False
 

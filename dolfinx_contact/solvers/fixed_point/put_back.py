@@ -44,4 +44,4 @@ def put_back(state: StepState, part: float) -> StepState:
         motion[:, :-1] = -nodes.slip_increment * (amount > part * largest)[:, None]
         contact.points.add_forces(motion, x)
     x[step.body.fixed] = state.x[step.body.fixed]
-    return step.evaluate(x, step.measuring_maps, c=state.c)
+    return step.evaluate(x, step.error_maps, c=state.c)

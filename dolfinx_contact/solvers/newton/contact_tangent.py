@@ -169,8 +169,8 @@ def next_change(state: StepState) -> float:
         return np.inf
     tangent = ContactTangent(body, [contact.points for contact in step.contacts])
     try:
-        near = step.evaluate(state.x, step.measuring_maps, before=state)
-        tangent.linearise(step.derivatives(near, step.measuring_maps))
+        near = step.evaluate(state.x, step.error_maps, before=state)
+        tangent.linearise(step.derivatives(near, step.error_maps))
         dx = tangent.solve(near.residual)
     except (LinearSolverError, PETSc.Error):
         return np.inf
