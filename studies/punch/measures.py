@@ -32,7 +32,7 @@ def zones(run: Run, step: int) -> Zones:
     a, b = disc.faces.ravel(), np.roll(disc.faces, -1, axis=1).ravel()
     both = stick[a] & stick[b]
     graph = coo_matrix((np.ones(both.sum()), (a[both], b[both])), shape=(len(stick),) * 2)
-    _, label = connected_components(graph, has_spatial_axes=False)
+    _, label = connected_components(graph, directed=False)
     rim, reverse = radius > RIM, disc.inward()
     return Zones(
         count=len(np.unique(label[stick])),
