@@ -202,7 +202,7 @@ def test_an_exception_while_ranks_book(scene, on, monkeypatch):
     assert run.is_(run.done)
 
 
-TOLD = ["warn_of_rounding", "warn_of_contact"]
+TOLD = ["warn_of_rounding", "warn_of_inaccurate_reactions"]
 
 
 @pytest.mark.ranks
