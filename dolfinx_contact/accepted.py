@@ -18,6 +18,7 @@ from dolfinx_contact.solvers.base import KEPT_STARTS
 
 if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import FreeState
+    from dolfinx_contact.bodies.internal_variables import InternalVariables
     from dolfinx_contact.contact.contact import Contact
     from dolfinx_contact.contact.state import History
     from dolfinx_contact.problem import ContactProblem
@@ -59,6 +60,16 @@ def poses_of(contacts: Sequence[Contact]) -> tuple[tuple, ...]:
     return tuple((*surface.stands[:2], surface.placed) for surface in surfaces)
 
 
+def histories_of(contacts: Sequence[Contact]) -> tuple[History, ...]:
+    """Return the history of each contact."""
+    return tuple(contact.history for contact in contacts)
+
+
+def values_of(internal: InternalVariables | None) -> tuple[np.ndarray, ...]:
+    """Return copies of the present values of internal variables; empty if there are none."""
+    return () if internal is None else internal.values()
+
+
 def put_surfaces(contacts: Sequence[Contact], poses: Sequence[tuple]) -> None:
     """Move each contact's surface to a pose returned by ``poses_of``."""
     for contact, (displacement, rotation, placed) in zip(contacts, poses):
@@ -71,8 +82,7 @@ def unloaded(problem: ContactProblem) -> Accepted:
     for contact in problem.contacts:
         contact.reset()
     zero = np.zeros(problem.body.size)
-    histories = tuple(contact.history for contact in problem.contacts)
-    values = problem.internal.values() if problem.internal else ()
+    histories, values = histories_of(problem.contacts), values_of(problem.internal)
     return Accepted(
         zero, zero, histories, poses_of(problem.contacts), None, values, (), problem.number
     )
@@ -89,7 +99,7 @@ def advanced(problem: ContactProblem, found: SolverResult) -> Accepted:
     histories = tuple(contact.ended(nodes, state.x) for contact, nodes in both)
     for contact in problem.contacts:
         contact.surface.end_step()
-    values = problem.internal.values() if problem.internal else ()
+    values = values_of(problem.internal)
     starts = before.starts if found.start is None else (*before.starts, found.start)[-KEPT_STARTS:]
     poses, free_state = poses_of(problem.contacts), problem.body.last_free_state
     return Accepted(state.x, before.x, histories, poses, free_state, values, starts, problem.number)
@@ -110,4 +120,4 @@ def show(problem: ContactProblem, accepted: Accepted) -> Accepted:
     body.show(accepted.x)
     if problem.internal:
         problem.internal.put(accepted.variables)
-    return accepted.replaced(histories=tuple(contact.history for contact in contacts))
+    return accepted.replaced(histories=histories_of(contacts))

@@ -17,7 +17,16 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from dolfinx_contact import compat
-from dolfinx_contact.accepted import Accepted, advanced, poses_of, put_surfaces, show, unloaded
+from dolfinx_contact.accepted import (
+    Accepted,
+    advanced,
+    histories_of,
+    poses_of,
+    put_surfaces,
+    show,
+    unloaded,
+    values_of,
+)
 from dolfinx_contact.checks.check import Check, CheckedStep, checked_checks, run_checks
 from dolfinx_contact.checks.scene import checks_of
 from dolfinx_contact.contact.contact import Contact
@@ -309,8 +318,7 @@ class ContactProblem(Guarded):
         Histories and internal variables that the user has changed since the last step are first
         stored in the accepted state.
         """
-        values = () if self.internal is None else self.internal.values()
-        histories = tuple(contact.history for contact in self.contacts)
+        histories, values = histories_of(self.contacts), values_of(self.internal)
         self._accepted = self._accepted.replaced(histories=histories, variables=values)
         return self._accepted, self._before, poses_of(self.contacts)
 

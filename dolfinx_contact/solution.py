@@ -118,11 +118,10 @@ def find(problem: ContactProblem, step: LoadStep, starts: Sequence[Any]) -> Solv
             return unmoved(step, statics.reason)
         if not statics.loads.any():
             found = floating(step)
-        pressed = np.concatenate([contact.last.reaction[:, -1] for contact in step.contacts])
-        if not body.largest(pressed) > 0.0:
-            statics.place()
-        else:
+        if step.was_held_by_contact:
             statics.follow()
+        else:
+            statics.place()
     elif not body.nonlinear:
         found = without_reactions(step)
     if found is None:

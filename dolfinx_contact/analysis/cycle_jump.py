@@ -154,29 +154,6 @@ def cycle_jump(
         >>> dc.cycle_jump(problem, cycle, 4).table[-1]["cycle"]
         4
     """
-    given = _start_or_continue(problem, cycle, cycles, accuracy, longest, max_cycles, path, monitor)
-    return _run_jumps(*given, monitor).result()
-
-
-def _start_or_continue(
-    problem: ContactProblem,
-    cycle: Any,
-    cycles: Any,
-    accuracy: Any,
-    longest: Any,
-    max_cycles: Any,
-    path: Any,
-    monitor: Any,
-) -> tuple:
-    """Check the arguments of ``cycle_jump``, and return the new or continued run.  Collective.
-
-    Returns:
-        The ``_Run``, the number of cycles, the largest number of cycles to simulate, and the
-        ``_Folder`` of checkpoints or None.
-
-    Raises:
-        ValueError: an argument is invalid, or the folder belongs to another run.
-    """
     comm = a_problem(problem).body.comm
     with raised_together(comm):
         cycles = int(positive("cycles", cycles, whole=True))
@@ -192,13 +169,14 @@ def _start_or_continue(
     if path is not None:
         folder = _Folder(path, run)
         folder.read(cycles)
-    return run, cycles, max_cycles, folder
+    _run_jumps(run, cycles, max_cycles, folder, monitor)
+    return run.result()
 
 
 def _run_jumps(
     run: _Run, cycles: int, most: int, folder: _Folder | None, monitor: Callable | None
-) -> _Run:
-    """Compute jumps until all cycles are completed, and return the run.  Collective.
+) -> None:
+    """Compute jumps until all cycles are completed.  Collective.
 
     In any case, also after an exception, the problem is left in the state at the end of the last
     jump.
@@ -222,7 +200,6 @@ def _run_jumps(
                 shown(run.record["done"])
         finally:
             run.restore_end()
-    return run
 
 
 def _check(problem: Any, cycle: object, monitor: object) -> None:

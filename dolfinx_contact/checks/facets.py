@@ -18,7 +18,7 @@ from mpi4py import MPI
 
 from dolfinx_contact.checks.check import NEGLIGIBLE_PART, Check, CheckedStep, place_of
 from dolfinx_contact.contact.contact import Contact
-from dolfinx_contact.contact.facets import Facets, facets_of, gauss
+from dolfinx_contact.contact.facets import Facets, gauss
 from dolfinx_contact.support.collective import raised_together
 
 # Unresolved length, relative to the largest ``r_n / kappa``, above which a warning is issued.
@@ -70,11 +70,6 @@ class Missed(NamedTuple):
         k = int(lengths.argmax())
         columns = (np.broadcast_to(column, lengths.shape)[k] for column in (size, needed, hollow))
         return max(self, Missed(float(lengths[k]), tuple(where[k].tolist()), *map(float, columns)))
-
-
-def facets_of_contact(contact: Contact) -> list[Facets]:
-    """Geometry of the facets of a contact, grouped by shape.  Collective."""
-    return facets_of(contact.displacements, contact.facets)
 
 
 class _FacetCheck(Check):

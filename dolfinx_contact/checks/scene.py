@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from dolfinx_contact.bodies.elastic import ElasticBody
     from dolfinx_contact.checks.growth import Turn
     from dolfinx_contact.contact.contact import Contact
+    from dolfinx_contact.contact.facets import Facets
     from dolfinx_contact.contact.interface import NodalStiffness
 
 # Mean strain above which the relative error of linear elasticity, half the strain, exceeds a tenth.
@@ -137,7 +138,7 @@ class Grows(Check):
         length = 0.5 * theta**2 * body.extent
         if theta <= NEGLIGIBLE_PART or length <= felt:
             return None
-        if length <= -body.highest(-np.concatenate([contact.present.gap for contact in contacts])):
+        if length <= smallest_gap(body, contacts):
             return None
         share = self._turn.share(contacts, u[: body.size], angles)
         if not (
@@ -191,7 +192,7 @@ class NothingTouches(Check):
 
 def smallest_gap(body: ElasticBody, contacts: Sequence[Contact]) -> float:
     """Smallest gap of all contact nodes on all ranks, length.  Collective."""
-    return -max(body.highest(-contact.present.gap) for contact in contacts)
+    return -body.highest(-np.concatenate([contact.present.gap for contact in contacts]))
 
 
 def _facing(body: ElasticBody, contact: Contact) -> float:
@@ -199,12 +200,15 @@ def _facing(body: ElasticBody, contact: Contact) -> float:
 
     It is positive if any facet faces the plane.  Collective.
     """
+    cosines = (-part.outwards @ contact.frame[-1] for part in _facets(contact))
+    return body.highest(np.concatenate([[-1.0], *cosines]))
+
+
+def _facets(contact: Contact) -> list[Facets]:
+    """Geometry of the facets of a contact, grouped by shape.  Collective."""
     from dolfinx_contact.contact.facets import facets_of
 
-    facets = facets_of(contact.displacements, contact.facets)
-    return body.highest(
-        np.concatenate([[-1.0], *(-part.outwards @ contact.frame[-1] for part in facets)])
-    )
+    return facets_of(contact.displacements, contact.facets)
 
 
 class NearestGap(Check):
@@ -275,7 +279,7 @@ def checks_of(body: ElasticBody, contacts: Sequence[Contact]) -> tuple[Check, ..
     if between:
         from dolfinx_contact.checks import facets
 
-        given = {contact: facets.facets_of_contact(contact) for contact in between}
+        given = {contact: _facets(contact) for contact in between}
         found += [facets.Straight(given), facets.Between(given)]
         wavy = [c for c in between if getattr(c.surface, "height", None) is not None]
         found += map(facets.Slopes, wavy)

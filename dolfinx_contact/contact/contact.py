@@ -280,8 +280,8 @@ class Contact(Guarded):
 
         See ``ContactStep.ended``.
         """
+        self._history, self._present = history, history.last
         self.laws.take(self, history.friction)
-        self.set_history(history)
         self.measure.renew(self)
 
     # -- results -------------------------------------------------------------------------------

@@ -389,7 +389,7 @@ class ContactStep:
         sums, worn, doubtful, worn_and_force = self._updated_sums(state)
         bare = None
         if geometry.renews_rows and u is not None:
-            bare = geometry.gap_at(u, frames)[1].alone
+            bare = geometry.projected(u, frames.left).points.alone
         ended = geometry.ended(frames)
         return History(
             state, ended, sums, self.friction, worn, bare, self.before, doubtful, worn_and_force

@@ -89,7 +89,7 @@ class MortarGeometry(NodalGeometry):
 
     @property
     def renews_rows(self) -> bool:
-        """See ``Geometry``."""
+        """See ``NodalGeometry``."""
         return self.surface.sliding == "large"
 
     def standing(self, depends_on_position: bool, before: Frames | None = None) -> Frames:
@@ -275,7 +275,7 @@ class MortarGeometry(NodalGeometry):
     def slip_past_edge(
         self, u: np.ndarray, frames: Frames, history: History
     ) -> tuple[np.ndarray, np.ndarray] | None:
-        """See ``Geometry``; the slip follows from the mortar rows at the start of the step."""
+        """See ``NodalGeometry``; the slip follows from the mortar rows at the start of the step."""
         if not frames.leaving:
             return None
         before, alone = history.frames, frames.points.alone
@@ -325,17 +325,17 @@ class MortarGeometry(NodalGeometry):
         )
 
     def on_all_ranks(self, worn: np.ndarray) -> np.ndarray:
-        """See ``Geometry``.  Collective."""
+        """See ``NodalGeometry``.  Collective."""
         return self._master.on_all_ranks(worn[:, None])[:, 0]
 
     def opened(self, points: MortarPoints, worn: np.ndarray | None) -> np.ndarray | None:
-        """See ``Geometry``."""
+        """See ``NodalGeometry``."""
         return None if worn is None else points.m @ worn
 
     def taken(
         self, volume: np.ndarray, area: np.ndarray, frames: Frames, history: History
     ) -> np.ndarray:
-        """See ``Geometry``: worn depths of the master nodes.  Collective.
+        """See ``NodalGeometry``: worn depths of the master nodes.  Collective.
 
         Node b loses the volume ``sum_a m_ab V_a``.  Negative volumes are set to zero and the others
         scaled, so that the total is kept.  Vertices of second-order triangles have no area; they
@@ -404,11 +404,11 @@ class MortarGeometry(NodalGeometry):
 
     @property
     def opposite(self) -> np.ndarray:
-        """See ``Geometry``."""
+        """See ``NodalGeometry``."""
         return self._master.nodes
 
     def covered(self, frames: Frames) -> np.ndarray:
-        """See ``Geometry``."""
+        """See ``NodalGeometry``."""
         return frames.points.share
 
     def slid(self, motion: np.ndarray, history: History) -> float:

@@ -135,7 +135,7 @@ class RigidGeometry(NodalGeometry):
         return self.x + moved - surface.point - surface.displacement
 
     def distances(self, x: np.ndarray) -> np.ndarray:
-        """See ``Geometry``."""
+        """See ``NodalGeometry``."""
         return self.surface.distances(x)
 
     def check_start(self, contact: Contact, body: ElasticBody) -> str:

@@ -19,7 +19,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from dolfinx_contact import compat
-from dolfinx_contact.accepted import Accepted, poses_of
+from dolfinx_contact.accepted import Accepted, histories_of, poses_of
 from dolfinx_contact.bodies.elastic import ElasticBody, FreeState
 from dolfinx_contact.contact.saved import check_saved, load_saved, saved_of
 from dolfinx_contact.contact.state import OPPOSITE_WEAR
@@ -191,7 +191,7 @@ def load(path: str | PathLike[str], problem: ContactProblem) -> Accepted:
     return problem.accepted.replaced(
         x=x,
         x_before=before,
-        histories=tuple(contact.history for contact in contacts),
+        histories=histories_of(contacts),
         poses=poses_of(contacts),
         free_state=_free_state(mine, comm),
         variables=internal.loaded(mine) if internal else (),

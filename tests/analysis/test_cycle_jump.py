@@ -131,12 +131,6 @@ def test_jumps_with_any_coefficient(power):
         assert found.volume == pytest.approx(approach, rel=ACCURACY)
 
 
-def in_order(contact):
-    """Worn depths of all nodes, along x."""
-    x, depth = (np.concatenate(COMM.allgather(a)) for a in (contact.x[:, 0], contact.wear_depth))
-    return depth[np.argsort(x)]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("power", [-12, -6, 0, 2, 4, 6])
 def test_partial_slip_with_any_coefficient(power):
@@ -149,7 +143,9 @@ def test_partial_slip_with_any_coefficient(power):
         cycle(done)
     scene, cycle = roller(coefficient, 2e-3)
     found = dc.cycle_jump(scene.problem, cycle, cycles, ACCURACY)
-    depth, true = (in_order(of.contact) for of in (scene, truth))  # ranks may share both otherwise
+    depth, true = (
+        scenes.by_position(of, "wear_depth") for of in (scene, truth)
+    )  # ranks may share both otherwise
     error = np.abs(depth - true).max() / true.max()
     assert found.reached and error <= ACCURACY / 2
     assert error <= max(3 * found.depth_error, ACCURACY / 100)
